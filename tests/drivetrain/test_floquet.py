@@ -196,3 +196,12 @@ def test_several_forces_that_other_modes_yield_to_by_direct_integration(damping:
     found = np.linalg.eigvals(monodromy(constant, edges, W, np.vstack([S, 0.0 * S]), strength(kick_times(edges)), R))
     assert (constant.values is None) == (damping[1] == 4.0)
     assert np.sort(np.abs(found)) == pytest.approx(np.sort(np.abs(expected)), rel=1e-7)
+
+
+def test_a_flow_of_one_freedom_serves_more_than_one_map() -> None:
+    """One pair of eigenvalues is a single row of coordinates, which is contiguous either way round."""
+    constant, edges = flow(np.array([[4.0]]), np.array([[0.1]]), 1.0), np.linspace(0.0, 1.0, 9)
+    strengths = -0.5 * np.cos(2.0 * math.pi * kick_times(edges))[..., None, None]
+    kicked = np.array([[1.0]]), np.array([[1.0], [0.0]]), strengths
+    first = monodromy(constant, edges, *kicked)
+    np.testing.assert_array_equal(monodromy(constant, edges, *kicked), first)

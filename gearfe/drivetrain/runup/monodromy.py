@@ -145,7 +145,7 @@ def monodromy(
     rows = (reads.T / np.concatenate([constant.scale, np.ones(n)])) @ constant.out
     length = (edges[-1] - edges[0]) / (len(edges) - 1)
     # columns of the map as rows, real and imaginary parts beside each other: products are real
-    x = np.ascontiguousarray(constant.into.T, dtype=complex)
+    x = np.array(constant.into.T, dtype=complex, order="C")  # a copy, which the kernel changes
     calm = constant.values is not None and length * float(np.abs(constant.values.real).max(initial=0.0)) < CALM
     begins, drifts = (PLACES, [*[0.0] * len(DRIFTS), 1.0]) if calm else (np.zeros(len(PLACES)), [*DRIFTS, 0.0])
     parts, width = _parts(x), 2 * x.shape[1]
