@@ -98,7 +98,9 @@ def _run_mesh(args: argparse.Namespace, mesh: NamedMesh) -> int:
         rows.append(_dynamic_factor(args.runup, train, mesh, rating))
     if args.with_computed:
         table = _with_computed(table, mesh, rows)
-        rating = rate_mesh(mesh, table, box.gears, box.meshes, pair)
+        sources = {"K_Hbeta": "from contact analysis", "K_v": "from the run-up"}
+        computed = {row.name: sources[row.name] for row in rows if row.name in sources}
+        rating = replace(rate_mesh(mesh, table, box.gears, box.meshes, pair), computed=computed)
     found: dict[str, Any] = rating_summary(rating, pair, table, mesh.name)
     if rows:
         found["computed"] = [row.row() for row in rows]

@@ -392,7 +392,11 @@ def _of_rating(results: Results) -> list[Sheet]:
         key=lambda row: wanted.index(row[0].partition(":")[0]) if row[0].partition(":")[0] in wanted else len(wanted)
     )
     edition = str(results.summary.get("edition", "ISO 6336"))
-    return [Sheet(f"Load capacity by {edition}", ("", *names, "unit"), rows, _warnings(results))]
+    start = [[str(cell) for cell in row] for row in (results.summary.get("basis") or ())[1:]]  # the first has the names
+    sheets = []
+    if start:
+        sheets.append(Sheet("Basis of the rating", ("", *names, "unit"), start, str(results.summary.get("method", ""))))
+    return [*sheets, Sheet(f"Load capacity by {edition}", ("", *names, "unit"), rows, _warnings(results))]
 
 
 def _cell(value: Any) -> str:

@@ -200,6 +200,9 @@ def test_computed_values_of_loads_along_the_width(tmp_path: Path) -> None:
     # the rating has the computed load factor, and the table that of the standard next to it
     assert rows["K_Hbeta"]["computed"] == made["influence"]["K_Hbeta"]["value"]
     assert rows["K_Hbeta"]["standard"] != rows["K_Hbeta"]["computed"]
+    assert made["influence"]["K_Hbeta"]["formula"] == "from contact analysis"
+    assert "K_Hβ from contact analysis" in made["method"]
+    assert all(0.0 <= rows[name]["error"] < 1.0 for name in roots)
     assert made["influence"]["K_Fbeta"]["value"] == pytest.approx(
         rows["K_Hbeta"]["computed"] ** made["influence"]["N_F"]["value"]
     )

@@ -26,6 +26,7 @@ from gearfe.gears.rating.load_factors import running_in, running_in_beta
 from gearfe.gears.rating.loss import loss
 from gearfe.gears.rating.materials import stress_number
 from gearfe.gears.rating.rate import Rating, rate, rate_mesh
+from gearfe.gears.rating.report import basis, method
 from gearfe.gears.rating.service import life_hours, miner
 from gearfe.gears.rating.stiffness import single_stiffness
 from tests.makers.rated import (
@@ -790,3 +791,31 @@ def test_pressure_of_the_fzg_pair_as_printed() -> None:
     ]
     rating = rate(MeshGeometry(gears[0], gears[1], 91.5e-3), {"torque_driver_Nm": 200.0, "speed_rpm": 1500.0})
     assert rating.flank.sigma_H0_MPa / rating.flank.Z_eps == pytest.approx(1347.3, abs=0.05)
+
+
+@pytest.mark.parametrize("drives", [0, 1])
+def test_basis_has_the_power_of_both_gears(drives: int) -> None:
+    """P = T omega of both gears is that of the driver's torque and speed, whichever gear drives."""
+    pair = spur_stage()
+    gears = (pair.pinion, pair.wheel) if drives == 0 else (pair.wheel, pair.pinion)
+    rating = rate(MeshGeometry(*gears, pair.wheel_centre), SPUR)
+    rows = {name: (one, two) for name, one, two, _ in basis(rating)}
+    mates = [float(text) for text in rows["mates that share the torque"]]
+    torque = SPUR["torque_driver_Nm"] / mates[rating.driver]
+    power = 1e-3 * torque * SPUR["speed_rpm"] * math.pi / 30.0
+    assert [float(text) for text in rows["power of this mesh"]] == pytest.approx([power, power], rel=1e-4)
+    assert float(rows["torque of this mesh"][rating.driver]) == pytest.approx(torque, rel=1e-4)
+
+
+def test_factors_that_are_not_the_standards_are_marked() -> None:
+    keys = SPUR | {"face_load_factor": 1.3}
+    rating = rate(spur_stage(), keys)
+    (row,) = [entry for entry in rating.entries() if entry.name == "K_Hbeta"]
+    assert row.formula == "prescribed"
+    assert "K_Hβ prescribed" in method(rating)
+    (row,) = [
+        entry
+        for entry in rate(spur_stage(), {key: keys[key] for key in keys if key != "face_load_factor"}).entries()
+        if entry.name == "K_Hbeta"
+    ]
+    assert row.formula.startswith("ISO 6336-1")

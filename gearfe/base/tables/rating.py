@@ -77,7 +77,7 @@ class GearRatingTable:
         None, low=0.0, doc="profile form deviation f_falpha (um), instead of that of quality"
     )
     helix_slope_um: float | None = quantity(
-        None, low=0.0, doc="helix slope deviation f_Hbeta (um), instead of that of quality"
+        None, low=0.0, doc="helix slope deviation f_Hbeta (um), instead of that of quality; no modification"
     )
     tip_relief_um: float | None = quantity(
         None,
@@ -183,7 +183,9 @@ class MeshRatingTable:
         None, above=0.0, high=1.0, doc="mean coefficient of friction; left out: from load, speed, oil and roughness"
     )
     misalignment_um: float | None = quantity(
-        None, low=0.0, doc="mesh misalignment of manufacture f_ma (um); left out: from both helix slope deviations"
+        None,
+        low=0.0,
+        doc="misalignment of manufacture f_ma (um), not that of [pair]; left out: from both helix slope deviations",
     )
     shaft_misalignment_um: float | None = quantity(
         None, low=0.0, doc="misalignment by deflection f_sh (um); left out: from the keys of the shaft, else 0"

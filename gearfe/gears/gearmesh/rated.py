@@ -33,13 +33,15 @@ POSITIONS, SINGLE = 24, 9
 
 @dataclass(frozen=True)
 class Compared:
-    """A value of the standard and the computed one."""
+    """A value of the standard and the computed one, with its estimated relative error where there is one."""
 
     name: str
     unit: str
     standard: float
     computed: float
     meaning: str
+    error: float | None = None
+    remark: str = ""
 
     @property
     def difference(self) -> float:
@@ -104,13 +106,25 @@ def _of_width(job: StiffnessJob, rating: Rating, torque: float) -> list[Compared
         standard = max(flank.Z_BD) * flank.sigma_H0_MPa * spread
         meaning = "largest contact stress, with K_Hbeta and K_Halpha; computed over the flanks, without edges"
         rows.append(Compared("largest pressure", "MPa", standard, 1e-6 * float(np.nanmax(pressure)), meaning))
-    stress = roots_of_cells(wide_roots(lines, sweep), sweep.status.shape).stress[0]
+    roots = wide_roots(lines, sweep)
+    cells = roots_of_cells(roots, sweep.status.shape)
+    stress = cells.stress[0]
+    ends = float(roots.z.min(axis=1).max()), float(roots.z.max(axis=1).min())
     for i, name in enumerate(rating.names):
         largest = stress[:, rating.of_pair[i]]
         if np.isfinite(largest).any():
             standard = rating.root.sigma_F0_MPa[i] * general.K_Fbeta * general.K_Falpha
             meaning = "largest root stress, with K_Fbeta and K_Falpha; computed over width and mesh cycle"
-            rows.append(Compared(f"root stress {name}", "MPa", standard, 1e-6 * float(np.nanmax(largest)), meaning))
+            at = int(np.nanargmax(largest))
+            error, place = (float(values[0, at, rating.of_pair[i]]) for values in (cells.error, cells.z))
+            remark = ""
+            if min(place - ends[0], ends[1] - place) < job.pair.pinion.module:
+                remark = (
+                    f"largest at y = {1e3 * place:.4g} mm, at the end of the face width: a loaded edge there gives a "
+                    "local stress, which is not the bending stress of ISO 6336-3"
+                )
+            largest_MPa = 1e-6 * float(largest[at])
+            rows.append(Compared(f"root stress {name}", "MPa", standard, largest_MPa, meaning, error, remark))
     return [row for row in rows if math.isfinite(row.computed)]
 
 
@@ -194,5 +208,8 @@ def compared_lines(rows: list[Compared]) -> list[str]:
         unit = "" if row.unit == "-" else f" {row.unit}"
         lines.append(
             f"  {row.name + unit:<26}{row.standard:>12.5g}{row.computed:>12.5g}{100.0 * row.difference:>+11.1f} %"
+            + ("" if row.error is None else f"  (estimated error {100.0 * row.error:.2g} %)")
         )
+        if row.remark:
+            lines.append(f"    {row.remark}")
     return lines

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ...base.config import build
@@ -52,6 +52,8 @@ class Rating(ShownTable):
         Factors of general influence; flanks; roots; life under the spectrum; loss factor.
     scuffing
         Temperatures of contact, None: without oil_temperature_C.
+    computed
+        Symbol -> computation that gave the factor instead of the standard.
     """
 
     edition: int
@@ -67,6 +69,19 @@ class Rating(ShownTable):
     service: Service
     loss: Loss
     scuffing: Scuffing | None
+    computed: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def sources(self) -> dict[str, str]:
+        """Symbol -> source of each factor K that is not the standard's."""
+        load, made = self.load, {}
+        if load.dynamic_factor is not None:
+            made["K_v"] = "prescribed"
+        if load.face_load_factor is not None:
+            made["K_Hbeta"] = "prescribed"
+        if load.transverse_load_factor is not None:
+            made |= dict.fromkeys(("K_Halpha", "K_Falpha"), "prescribed")
+        return made | dict(self.computed)
 
     @property
     def S_H(self) -> tuple[float, float]:
@@ -89,7 +104,14 @@ class Rating(ShownTable):
         groups["loss"] = self.loss
         if self.scuffing is not None:
             groups["scuffing"] = self.scuffing
-        return [entry for group, results in groups.items() for entry in entries(group, results)]
+        made = [entry for group, results in groups.items() for entry in entries(group, results)]
+        sources = self.sources
+        return [
+            replace(row, formula=sources[row.name], meaning=f"{row.meaning} ({sources[row.name]})")
+            if row.group == "influence" and row.name in sources
+            else row
+            for row in made
+        ]
 
     def facts(self) -> Mapping[str, str]:
         """Edition, safety factors."""

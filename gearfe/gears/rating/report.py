@@ -56,6 +56,8 @@ def rating_summary(rating: Rating, pair: GearPair, table: RatingTable, mesh: str
         "edition": f"ISO 6336:{rating.edition}",
         "gears": dict(zip(("gear_1", "gear_2"), rating.names, strict=True)),
         "driver": names[0],
+        "method": method(rating),
+        "basis": [list(row) for row in basis(rating)],
         "safety": {
             symbol: dict(zip(rating.names, values, strict=True))
             for symbol, values in (("S_H", rating.S_H), ("S_F", rating.S_F))
@@ -200,9 +202,60 @@ PRINTED = {
 }
 
 
+def method(rating: Rating) -> str:
+    """Return the edition, the methods, and the edition of the formula numbers."""
+    face = rating.sources.get("K_Hbeta", "by method C")
+    return f"ISO 6336:{rating.edition}, method B, K_Hβ {face}; formula numbers of the edition of 2006"
+
+
+def basis(rating: Rating) -> list[tuple[str, str, str, str]]:
+    """Return what a rating starts from: name, value of gear 1, value of gear 2 and unit of each row."""
+    general, load, pair = rating.general, rating.load, rating.pair
+    one, two = rating.strengths
+    torques = [0.5e-3 * general.F_t_N * abs(d) for d in pair.d]
+    turns = load.speed * (abs(pair.u) if rating.driver else 1.0)
+    speeds = turns, turns / abs(pair.u)
+    roles = ["driver" if i == rating.driver else "driven" for i in (0, 1)]
+
+    def both(*values: float | None) -> tuple[str, str]:
+        texts = ["-" if value is None else f"{value:.5g}" for value in values]
+        return texts[0], texts[-1]
+
+    rows: list[tuple[str, str, str, str]] = [
+        ("gear", *rating.names, ""),
+        ("role", roles[0], roles[1], ""),
+        ("teeth", *both(*pair.z), ""),
+        ("torque of this mesh", *both(*torques), "N m"),
+        ("mates that share the torque", *both(one.mates, two.mates), ""),
+        ("speed", *both(*speeds), "1/min"),
+        (
+            "power of this mesh",
+            *both(*(1e-3 * t * n * math.pi / 30.0 for t, n in zip(torques, speeds, strict=True))),
+            "kW",
+        ),
+        ("common face width", *both(pair.b), "mm"),
+        ("material", one.material, two.material, ""),
+        ("hardness", *both(one.brinell, two.brinell), "HBW"),
+        ("σ_Hlim", *both(one.sigma_H_lim, two.sigma_H_lim), "MPa"),
+        ("σ_Flim", *both(one.sigma_F_lim, two.sigma_F_lim), "MPa"),
+        ("flank tolerance class, ISO 1328-1", *both(one.quality, two.quality), ""),
+        ("application factor K_A", *both(general.K_A), ""),
+        ("required life", *both(load.hours), "h"),
+        ("oil viscosity at 40 °C", *both(load.viscosity_40), "mm²/s"),
+        ("required S_Hmin", *both(load.flank_safety), ""),
+        ("required S_Fmin", *both(load.root_safety), ""),
+    ]
+    if load.oil is not None:
+        rows.append(("required safety against scuffing", *both(load.scuffing_safety), ""))
+    if "K_Hbeta" not in rating.sources and load.shaft_misalignment is None and load.bearing_span is None:
+        rows.append(("f_sh (no data of the pinion's shaft)", *both(0.0), "µm"))
+    return rows
+
+
 def rating_lines(rating: Rating) -> list[str]:
-    """Lines to print: the main values of both gears."""
-    lines = [f"ISO 6336:{rating.edition}, method B: {rating.names[0]} (gear 1), {rating.names[1]} (gear 2)"]
+    """Lines to print: the basis and the main values of both gears."""
+    lines = [method(rating)]
+    lines += [f"  {name:<36}{one:>12}  {two:>12}  {unit}".rstrip() for name, one, two, unit in basis(rating)]
     for entry in rating.entries():
         if entry.name in PRINTED[entry.group]:
             pair = entry.value if isinstance(entry.value, tuple) else (entry.value,)
