@@ -115,6 +115,33 @@ def test_another_compiler_or_processor_needs_kernels_of_its_own(
     assert compiled.cache_folder((compiled.interpreted,)) != here
 
 
+def test_constants_of_other_modules_are_in_the_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Numbers, enumerations and arrays that are compiled in; a tuple of functions differs from process to process."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "using_kernels.py").write_text(
+        "from other_constants import CODE, KIND, TABLE, CALLS\n"
+        "def f(x):\n    return x * CODE + KIND.one.value + TABLE[0] + CALLS[0](x)\n"
+    )
+    keys = []
+    for code, kind, table in ((1, 1, 1.0), (1, 1, 1.0), (2, 1, 1.0), (1, 2, 1.0), (1, 1, 2.0)):
+        (tmp_path / "other_constants.py").write_text(
+            "from enum import Enum\nimport numpy as np\n"
+            f"CODE = {code}\nTABLE = np.array([{table}])\nCALLS = (lambda x: x,)\n"
+            f"class KIND(Enum):\n    one = {kind}\n"
+        )
+        script = (
+            "import sys, using_kernels as u\nfrom gearfe.multibody.compiled import kernels\n"
+            "print(kernels._key((u.f,), ()))"
+        )
+        made = subprocess.run(
+            [sys.executable, "-B", "-c", script], cwd=tmp_path, env={**os.environ, "PYTHONPATH": f"{tmp_path}:{ROOT}"},
+            check=True, capture_output=True, text=True,
+        )  # fmt: skip
+        keys.append(made.stdout)
+    assert keys[0] == keys[1]
+    assert len(set(keys)) == 4
+
+
 @pytest.mark.slow
 def test_a_command_compiles_them(tmp_path: Path) -> None:
     """The first run says that it compiles; one after the command does not."""

@@ -20,6 +20,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from types import FunctionType, SimpleNamespace
@@ -87,11 +88,31 @@ def _key(functions: tuple[Callable[..., Any], ...], options: tuple[str, ...]) ->
 
 
 def _text(functions: Iterable[Callable[..., Any]]) -> str:
-    """Names of the functions, and the modules that hold them."""
+    """Names of the functions, the modules that hold them, and the constants that are compiled in from other modules."""
     functions = tuple(functions)
     files = dict.fromkeys(f.__code__.co_filename for f in functions if isinstance(f, FunctionType))
     names = [f"# {f.__module__}.{f.__qualname__}" for f in functions]
-    return "\n".join([*names, *(Path(file).read_text(encoding="utf-8") for file in files)])
+    return "\n".join([*names, *_constants(functions), *(Path(file).read_text(encoding="utf-8") for file in files)])
+
+
+def _constants(functions: Iterable[Callable[..., Any]]) -> Iterator[str]:
+    """Return the global numbers, texts, arrays and enumerations that the functions use, with their values."""
+    for f in functions:
+        used = f.__code__.co_names if isinstance(f, FunctionType) else ()
+        for name in used:
+            value: Any = f.__globals__.get(name)
+            if isinstance(value, type) and issubclass(value, Enum):
+                value = [(member.name, member.value) for member in value]
+            elif hasattr(value, "tobytes"):
+                value = value.dtype.str, value.shape, value.tobytes()
+            elif not _plain(value):
+                continue
+            yield f"# {f.__qualname__}: {name} = {value!r}"
+
+
+def _plain(value: Any) -> bool:
+    """Whether a value is a number, a text or a tuple of such, whose text is the same in every process."""
+    return isinstance(value, int | float | complex | str) or (isinstance(value, tuple) and all(map(_plain, value)))
 
 
 def _roots() -> list[Path]:
