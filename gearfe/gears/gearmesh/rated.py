@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...base.errors import given
+from ...base.shown import percent
 from ..contact.laws import PairModel, check_torque
 from ..rating.rate import Rating
 from ..width import sweep_width
@@ -208,7 +209,7 @@ def compared_lines(rows: list[Compared]) -> list[str]:
         unit = "" if row.unit == "-" else f" {row.unit}"
         lines.append(
             f"  {row.name + unit:<26}{row.standard:>12.5g}{row.computed:>12.5g}{100.0 * row.difference:>+11.1f} %"
-            + ("" if row.error is None else f"  (estimated error {100.0 * row.error:.2g} %)")
+            + ("" if row.error is None else f"  (estimated error {percent(row.error)})")
         )
         if row.remark:
             lines.append(f"    {row.remark}")
