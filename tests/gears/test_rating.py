@@ -669,7 +669,10 @@ def test_a_rating_shows_itself() -> None:
     assert "S_H 1.21/1.377" in repr(rating)
     columns = rating.columns()
     assert len({len(list(values)) for values in columns.values()}) == 1
-    assert all("ISO" in text for text in columns["formula"])
+    sources = zip(columns["name"], columns["formula"], strict=True)
+    assert {name: text for name, text in sources if "ISO" not in text} == dict.fromkeys(
+        ("K_v", "K_Hbeta"), "prescribed"
+    )
     assert any("below the required 1.25" in sentence for sentence in rating.warnings)
 
 
