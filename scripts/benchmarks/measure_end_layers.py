@@ -99,7 +99,7 @@ def write(folder: Path, crowning: float, size: float) -> None:
     text = text.replace(kind + one, "".join(f"{kind}{name}, S_pinion_contact\n" for name in names))
     text = text.replace("*BOUNDARY\n", "*BOUNDARY\n" + "".join(f"{node}, 3, 3\n" for node in middle), 1)
     printed = "".join(f"*CONTACT PRINT, SLAVE={name}, MASTER=S_pinion_contact\nCF\n" for name in names)
-    deck.write_text(text[: text.index("*NODE PRINT")] + printed + "*END STEP\n", encoding="ascii")
+    deck.write_text(text[: text.index("*NODE PRINT")] + printed + "*END STEP\n", encoding="ascii", newline="\n")
     z = np.linspace(levels[0], high, 400001)
     order = np.argsort(points.z)
     load = np.interp(z, points.z[order], points.line_load[order], left=0.0, right=0.0)
