@@ -271,8 +271,9 @@ def test_choosing_positions(gears, elastic):
     curve: StiffnessCurve = sweep_stiffness(gears, twist=TWIST, angles=np.radians([1.0, 2.0, 3.0]), elastic=elastic)
     assert list(chosen_positions(curve, [3.0, 1.0, 3.0])) == [0, 2]
     assert list(chosen_positions(curve, None)) == [0, 1, 2]
-    with pytest.raises(InputError, match=r"none of the sweep's angles; the nearest is 3 deg"):
-        chosen_positions(curve, [3.4])
+    assert list(chosen_positions(curve, [1.6, 3.4])) == [1, 2]  # the nearest
+    with pytest.raises(InputError, match=r"is outside of the computed pinion angles; the nearest is 3 deg"):
+        chosen_positions(curve, [4.1])
 
 
 def test_the_size_is_told_before(elastic):
