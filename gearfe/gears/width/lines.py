@@ -519,7 +519,7 @@ class Placing:
     column: IntArray
     keys: IntArray
     loads: list[Array]
-    stretches: Stretches
+    stretches: Runs
 
     def flat(self, values: Array) -> Array:
         """Return the values of all points, shape (q,), of those by position, shape (m, n)."""
@@ -551,7 +551,7 @@ def place_points(
     """
     mesh, law, (cycle, turn) = lines.compliance.mesh, lines.law, _pitches(lines.compliance.mesh)
     stretches = _stretches(looks, runs, LEAST_STRETCH * mesh.width)
-    middle, half = 0.5 * (stretches.low + stretches.high), 0.5 * (stretches.high - stretches.low)
+    middle, half = 0.5 * (stretches.start + stretches.end), 0.5 * (stretches.end - stretches.start)
     counts = np.ceil(lines.density * mesh.count * np.sqrt(2.0 * half / mesh.width) - 1e-9).astype(np.int64)
     counts = np.maximum(LEAST_POINTS, counts)
     x, weight = np.concatenate([np.zeros((2, 0)), *(_gauss(count) for count in counts.tolist())], axis=1)
@@ -581,26 +581,8 @@ def place_points(
     return Placing(chosen, twist[chosen], points, count, row, column, keys, loads, stretches)
 
 
-@dataclass(frozen=True)
-class Stretches:
-    """Stretches of the loaded parts between kinks, s of them, by position, tooth pair and z.
-
-    Attributes
-    ----------
-    position, pair : ndarray, shape (s,)
-        Numbers of the positions, and tooth pairs.
-    low, high : ndarray, shape (s,)
-        Between which z (m).
-    """
-
-    position: IntArray
-    pair: IntArray
-    low: Array
-    high: Array
-
-
-def _stretches(looks: Looks, runs: Runs, least: float) -> Stretches:
-    """Divide runs at kinks that are `least` (m) apart."""
+def _stretches(looks: Looks, runs: Runs, least: float) -> Runs:
+    """Divide runs at kinks that are `least` (m) apart, in the order of positions, tooth pairs and z."""
     z, keys = looks.z[looks.kink], _keys(looks.position, looks.pair)[looks.kink]
     order = np.lexsort((np.concatenate([runs.start, z]), np.concatenate([runs.keys, keys])))
     run = np.empty(len(order), dtype=np.int64)
@@ -615,7 +597,7 @@ def _stretches(looks: Looks, runs: Runs, least: float) -> Stretches:
     low, high = np.concatenate([runs.start, z]), np.concatenate([runs.end, z])
     run = np.sort(of_run)
     low, high = low[np.lexsort((low, of_run))], high[np.lexsort((high, of_run))]
-    return Stretches(runs.position[run], runs.pair[run], low, high)
+    return Runs(runs.position[run], runs.pair[run], low, high)
 
 
 @cache
@@ -874,7 +856,7 @@ class Solution:
     wheel_moment: Array
     tangent: Array
     placed: float
-    stretches: Stretches
+    stretches: Runs
     converged: bool
     steps: int
     placings: int
@@ -931,16 +913,16 @@ def _line_loads(lines: ContactLines, angle: Array, solutions: Sequence[Solution]
     """Line loads of a batch of positions, of which the first has a number."""
     mesh, numbers = lines.compliance.mesh, np.arange(len(solutions))
     parts = joined([replace(one.stretches, position=one.stretches.position + i) for i, one in enumerate(solutions)])
-    keys = _keys(parts.position, parts.pair)
-    begins = np.append(True, (np.diff(keys) > 0) | (parts.low[1:] != parts.high[:-1]))[: len(keys)]
+    begins = np.append(True, (np.diff(parts.keys) > 0) | (parts.start[1:] != parts.end[:-1]))[: len(parts.pair)]
     run = np.cumsum(begins) - 1
-    whole = (np.bincount(run, parts.high - parts.low))[run]
-    counts = np.maximum(LEAST_DENSE, np.ceil(DENSE * np.sqrt((parts.high - parts.low) / whole)).astype(np.int64))
+    length = parts.end - parts.start
+    share_of_run = length / np.bincount(run, length)[run]
+    counts = np.maximum(LEAST_DENSE, np.ceil(DENSE * np.sqrt(share_of_run)).astype(np.int64))
     # a kink once
     share = [_dense(count)[0 if begin else 1 :] for count, begin in zip(counts.tolist(), begins.tolist(), strict=True)]
     of, x = np.repeat(np.arange(len(share)), [len(one) for one in share]), np.concatenate([np.zeros(0), *share])
     placed, twist = (np.array([getattr(one, name) for one in solutions]) for name in ("placed", "twist"))
-    middle, z = _middle(lines, angle, placed), parts.low[of] + (parts.high - parts.low)[of] * x
+    middle, z = _middle(lines, angle, placed), parts.start[of] + length[of] * x
     looks = _looks(lines, middle, np.zeros(len(middle)), parts.position[of], parts.pair[of], z, (x == 0.0) | (x == 1.0))
 
     points = joined([replace(one.points, influence=np.zeros((len(one.points), 0))) for one in solutions])
