@@ -26,7 +26,7 @@ CASES: tuple[tuple[str, Any, dict[str, Any], dict[str, str]], ...] = (
     (
         "helical stage, R_a1 R_a2 and B_M 13.795",
         rated.helical_stage,
-        rated.HELICAL | rated.HELICAL_OIL | rated.HELICAL_FLASH,
+        rated.helical_flash(),
         rated.HELICAL_FLASH_PRINTED,
     ),
     ("planet and ring", rated.spur_ring, rated.SPUR_RING, rated.SPUR_RING_PRINTED),

@@ -119,7 +119,7 @@ def test_planets_that_overlap_are_named() -> None:
 
 
 def test_gears_that_overlap_without_a_carrier_are_listed() -> None:
-    """What stands in a drawing may not fit yet."""
+    """A drawing may show gears that do not fit yet."""
     raw = tomllib.loads(text())
     raw["shafts"]["s3"]["x_mm"] = raw["shafts"]["s1"]["x_mm"] + 1.0
     layout = gearbox_layout(raw, "box.toml")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from gearfe import Gear
+from gearfe import Gear, rate
 from gearfe.gears.geometry.curves import inv
 from gearfe.gears.geometry.mesh_geometry import MeshGeometry
 
@@ -401,13 +401,23 @@ HELICAL_SCUFFING_LOOSE: dict[str, str] = {
     "theta_MC_C": "91.37",
     "mu_m": "0.041",
 }
-#: What all printed flash temperatures have in common: X_R twice in the friction, as if R_a were the product of both
-#: roughnesses, B_M 13.795 for the printed 13.780, and w_Bt as printed, by K_v.
-HELICAL_FLASH: dict[str, Any] = {
-    "friction_coefficient": 0.046542283 * 0.6**0.25,
-    "thermal_contact_N_per_mm_m05_s05_K": 13.795,
-    "dynamic_factor": 1.092409776 * 1119.632 / 1119.6836,
-}
+
+
+def helical_flash() -> dict[str, Any]:
+    """Return what all printed flash temperatures of the helical stage have in common, as keys of its rating.
+
+    These are X_R = 0.6^0.25 twice in the friction, as if R_a were the product of both roughnesses, B_M 13.795 for the
+    printed 13.780, and w_Bt as printed, by K_v.
+    """
+    rating = rate(helical_stage(), HELICAL | HELICAL_OIL)
+    assert rating.scuffing is not None
+    return HELICAL | HELICAL_OIL | {
+        "friction_coefficient": rating.scuffing.mu_m * 0.6**0.25,
+        "thermal_contact_N_per_mm_m05_s05_K": 13.795,
+        "dynamic_factor": rating.general.K_v * 1119.632 / rating.scuffing.w_Bt_N_per_mm,
+    }  # fmt: skip
+
+
 HELICAL_FLASH_PRINTED: dict[str, str] = {
     "mu_m": "0.041",
     "theta_flm_K": "30.20",

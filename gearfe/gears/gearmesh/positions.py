@@ -27,8 +27,8 @@ no mesh. From the truth they are as far as from that, and that from the truth, a
 What a law yields by itself (the overlap of a soft penalty) is in it.
 
 Not in it are the errors of the model (plane, no friction, rigid bores, small strain with its first-order correction),
-and errors that no refinement of one mesh family shows. In the half-plane law that is the wedge in place of a sharp tip,
-0.2 to 0.4 % where a tip carries load (docs/contact_laws.md). `scripts/benchmarks/measure_curve_accuracy.py` measures
+and errors that no refinement of one mesh family shows. In the half-plane law that is the wedge at a sharp tip, 0.2
+to 0.4 % where a tip carries load (docs/contact_laws.md). `scripts/benchmarks/measure_curve_accuracy.py` measures
 over random pairs how often it covers the true error.
 """
 
